@@ -71,6 +71,9 @@ class Inbox {
   [[nodiscard]] bool stop_waits() const noexcept {
     return (urgent_.load(std::memory_order_relaxed) & (kStop0 | kStop1 | kStop2)) != 0;
   }
+  /// Whether the last cycle is over. What confirmed() then lacks no cycle carries out: ask this
+  /// first.
+  [[nodiscard]] bool closed() const noexcept { return closed_.load(std::memory_order_acquire); }
   /// The number of the cycle that has carried out the stop `number`; empty: none has yet. A loop
   /// that hangs never does. Not more than 2^23 stops later.
   [[nodiscard]] std::optional<std::uint64_t> confirmed(std::uint32_t number) const noexcept {
@@ -137,6 +140,8 @@ class Inbox {
     confirmed_cycle_.store(cycle, std::memory_order_relaxed);
     confirmed_.store(taken_, std::memory_order_release);
   }
+  /// After the last confirm().
+  void close() noexcept TANDEM_RT { closed_.store(true, std::memory_order_release); }
   [[nodiscard]] std::optional<CycleRequest> take_request() noexcept TANDEM_RT {
     return get<CycleRequest>(requests_);
   }
@@ -185,6 +190,7 @@ class Inbox {
   std::atomic<std::uint64_t> reset_known_{kNow};
   std::atomic<std::uint32_t> confirmed_{0};
   std::atomic<std::uint64_t> confirmed_cycle_{0};
+  std::atomic<bool> closed_{false};
   static_assert(std::atomic<std::uint32_t>::is_always_lock_free);
 
   SpscRing requests_{sizeof(CycleRequest), kCapacity};

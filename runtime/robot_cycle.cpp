@@ -383,7 +383,10 @@ void RobotCycle::write() noexcept TANDEM_RT {
 void RobotCycle::hand_over() noexcept TANDEM_RT {
   shown_.take();
   if (now_.events != nullptr) now_.events->take(shown_.view());
-  if (!now_.outside.closed) now_.inbox.confirm(now_.time.cycle);
+  if (!now_.outside.closed) {
+    now_.inbox.confirm(now_.time.cycle);
+    if (now_.run.in(RunPhase::kDone)) now_.inbox.close();
+  }
   const std::int64_t now_ns = now_.loop.finish();
   now_.controllers.shadows().note_end_of_cycle(now_ns);
   took_ns_ = now_ns - now_.tick.begin_ns + std::max<std::int64_t>(now_.tick.wakeup_ns, 0);

@@ -120,6 +120,7 @@ Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCate
   const auto deadline = SteadyClock::now() + patience;
   Json answer{{"category", hal::to_string(category)}, {"paused", false}, {"confirmed", true}};
   for (;;) {
+    const bool over = cycle.inbox().closed();  // before: its last cycle confirms, and then closes
     if (const auto carried_out = cycle.inbox().confirmed(number)) {
       answer["cycle"] = *carried_out;
       answer["category"] = hal::to_string(carried_out_category(cycle, *carried_out, category));
@@ -130,9 +131,7 @@ Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCate
       answer["confirmed"] = false;
       return answer;
     }
-    if (cycle.progress().phase.load() == runtime::RunPhase::kDone) {
-      return fail("the run is over: its loop stops nothing any more");
-    }
+    if (over) return fail("the run is over: its loop stops nothing any more");
     if (SteadyClock::now() > deadline) break;
     std::this_thread::sleep_for(kLook);
   }

@@ -79,12 +79,14 @@ ControlRegistry::Gate gate_of(const runtime::RemoteOptions& remote, const remote
 /// A run, or a server: the loop and all that talks to it. Taken apart in reverse order.
 class Session {
  public:
+  /// @param listener  of the wait for its start; null: it did not wait
   Session(WiredComposition& composition, const RunOptions& options, Gate* gate,
-          ServiceNotice& notice)
+          ServiceNotice& notice, std::unique_ptr<ControlListener> listener)
       : c_(composition),
         options_(options),
         gate_(gate),
         notice_(notice),
+        listener_(std::move(listener)),
         out_(human_output(options.json)),
         admission_(composition.experiment.remote.trust == runtime::RemoteTrust::kDomain) {}
 
@@ -126,6 +128,14 @@ class Session {
     const std::vector<std::string> faults = latched_texts(cycle_->faults());
     return faults.empty() ? std::string() : faults.front();
   }
+  /// What it leaves to the wait for its start, from which on it answers nobody.
+  [[nodiscard]] StartRoom::Before end() {
+    auto listener = ControlSocket::end(std::move(socket_));
+    if (cycle_->inbox().stop_waits()) rt::request_emergency_stop();  // which no cycle has seen
+    return {not_enabled(), stopped(), std::move(listener)};
+  }
+
+ private:
   /// A person's emergency stop that is latched.
   [[nodiscard]] std::optional<runtime::FaultReport> stopped() const {
     for (runtime::FaultReport& fault : cycle_->faults()) {
@@ -135,8 +145,6 @@ class Session {
     }
     return std::nullopt;
   }
-
- private:
   [[nodiscard]] const runtime::Experiment& experiment() const { return c_.experiment; }
   /// This process in ROS 2's graph.
   [[nodiscard]] const char* node() const { return options_.serves ? "tandem_serve" : "tandem_run"; }
@@ -243,7 +251,8 @@ class Session {
     auto socket = serve(commands_, {.path = options_.socket,
                                     .kind = "run",
                                     .wanted = !options_.no_socket,
-                                    .needed = on_robot});
+                                    .needed = on_robot,
+                                    .listener = std::move(listener_)});
     if (!socket) return std::unexpected(socket.error());
     socket_ = std::move(*socket);
     if (server_ != nullptr && socket_ == nullptr &&
@@ -365,6 +374,7 @@ class Session {
   const RunOptions& options_;
   Gate* const gate_;  // null: without --gate
   ServiceNotice& notice_;
+  std::unique_ptr<ControlListener> listener_;  // until the socket serves
   std::FILE* out_;
   std::size_t plugins_at_start_ = 0;  // in the log's first record
   std::unique_ptr<DdsRun> dds_;
@@ -402,9 +412,10 @@ void warn_of_inertias(const runtime::Experiment& e) {
 }
 
 /// Connects to the robot; before, with --wait-for-start, waits until somebody asks for it.
+/// @param listens  set: where who asks waits for the run
 /// @return nothing: it is connected. Else with what the process ends
 std::optional<Exit> reach(WiredComposition& c, const RunOptions& options, ServiceNotice& notice,
-                          const StartRoom::Before& before) {
+                          StartRoom::Before before, std::unique_ptr<ControlListener>& listens) {
   if (!options.waits_for_start) {
     const Diagnostics errors = connect(c, options.record_frames);
     return errors.empty() ? std::nullopt : std::optional(refuse(errors));
@@ -415,7 +426,8 @@ std::optional<Exit> reach(WiredComposition& c, const RunOptions& options, Servic
                        "leave --wait-for-start out, and give it to `tandem serve`")
                       .error());
   }
-  auto room = StartRoom::open(options.socket, notice, before, c.experiment.robot.emergency_stop);
+  auto room =
+      StartRoom::open(options.socket, notice, std::move(before), c.experiment.robot.emergency_stop);
   if (!room) return refuse(room.error());
   for (;;) {
     if (!(*room)->await()) {
@@ -426,7 +438,10 @@ std::optional<Exit> reach(WiredComposition& c, const RunOptions& options, Servic
     if (errors.empty() && !options.no_log) {
       if (Status log = runtime::make_log_room(c, options.log_folder); !log) errors = {log.error()};
     }
-    if ((*room)->answer(errors.empty() ? std::nullopt : std::optional(errors.front()))) return {};
+    if ((*room)->answer(errors.empty() ? std::nullopt : std::optional(errors.front()))) {
+      listens = (*room)->end();
+      return {};
+    }
     disconnect(c);
   }
 }
@@ -447,15 +462,17 @@ Exit run_once(RunOptions options, Gate* gate, ServiceNotice& notice, ReportOfRun
   outlive_files();
   if (const Diagnostics errors = check_events((*composition)->experiment); !errors.empty())
     return refuse(errors);
-  if (const auto ended = reach(**composition, options, notice, std::exchange(again, {})))
+  std::unique_ptr<ControlListener> listens;
+  if (const auto ended = reach(**composition, options, notice, std::exchange(again, {}), listens))
     return *ended;
   print_warnings((*composition)->warnings);
   set_pace(**composition, options);
   if (const Status paced = check_pace(**composition, options); !paced) return refuse(paced.error());
   note_overrun_policy(**composition, options);
-  auto session = std::make_unique<Session>(**composition, options, gate, notice);
+  auto session =
+      std::make_unique<Session>(**composition, options, gate, notice, std::move(listens));
   const Exit exit = session->run();
-  if (session->waits_again()) again = {session->not_enabled(), session->stopped()};
+  if (session->waits_again()) again = session->end();
   if (options.report) {
     report = {session->log(), session->log_is_whole(),
               options.quiet ? nullptr : human_output(options.json)};

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <thread>
 #include <utility>
 
 #include "apps/control/fault_table.hpp"
@@ -15,7 +14,6 @@ namespace tandem::apps {
 namespace {
 
 constexpr std::chrono::milliseconds kLook{50};  // between two looks for a signal
-constexpr std::chrono::milliseconds kOut{100};  // for an answer to leave before the socket closes
 constexpr char kWaits[] = "waits for its start: tandem controller start";
 constexpr char kStopped[] =
     "waits, and an emergency stop is latched: tandem fault reset, then tandem controller start";
@@ -30,13 +28,15 @@ hal::StopCategory retreatless(hal::StopCategory category) {
 }  // namespace
 
 Result<std::unique_ptr<StartRoom>> StartRoom::open(const std::string& socket, ServiceNotice& notice,
-                                                   const Before& before,
-                                                   hal::StopCategory declared) {
+                                                   Before before, hal::StopCategory declared) {
   std::unique_ptr<StartRoom> room(new StartRoom(notice, declared));
   room->stop_ = before.stop;
   room->add_commands();
-  auto opened =
-      serve(room->commands_, {.path = socket, .kind = "run", .wanted = true, .needed = true});
+  auto opened = serve(room->commands_, {.path = socket,
+                                        .kind = "run",
+                                        .wanted = true,
+                                        .needed = true,
+                                        .listener = std::move(before.listener)});
   if (!opened) return std::unexpected(opened.error());
   room->socket_ = std::move(*opened);
   rt::install_emergency_signal();
@@ -169,8 +169,6 @@ bool StartRoom::await() {
     if (rt::stop_requested()) ends_ = true;
     if (ends_) {
       news_.notify_all();
-      lock.unlock();
-      std::this_thread::sleep_for(kOut);
       return false;
     }
     if (wanted_) return true;
@@ -191,12 +189,8 @@ bool StartRoom::answer(std::optional<Error> refused) {
     ++answers_;
   }
   news_.notify_all();
-  if (refused) {
-    tell(refused->to_string());
-    return false;
-  }
-  std::this_thread::sleep_for(kOut);
-  return true;
+  if (refused) tell(refused->to_string());
+  return !refused;
 }
 
 }  // namespace tandem::apps

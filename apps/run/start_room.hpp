@@ -25,14 +25,14 @@ class StartRoom {
  public:
   /// Why it waits again.
   struct Before {
-    std::string why{};                           ///< empty: it waits for the first time
-    std::optional<runtime::FaultReport> stop{};  ///< an emergency stop, which stays latched
+    std::string why{};                            ///< empty: it waits for the first time
+    std::optional<runtime::FaultReport> stop{};   ///< an emergency stop, which stays latched
+    std::unique_ptr<ControlListener> listener{};  ///< of the run; null: it waits for the first time
   };
   /// @param declared  the robot's emergency stop
   /// Errors: apps::serve()'s of a socket that is needed.
   [[nodiscard]] static Result<std::unique_ptr<StartRoom>> open(const std::string& socket,
-                                                               ServiceNotice& notice,
-                                                               const Before& before,
+                                                               ServiceNotice& notice, Before before,
                                                                hal::StopCategory declared);
 
   /// Blocks until somebody asks for the start. @return false: for the run's end instead, by a
@@ -42,6 +42,10 @@ class StartRoom {
   /// @return whether the run goes on to its robot. Else it waits on: it was refused, or an
   /// emergency stop came meanwhile. A stop that comes later is the first thing that the run sees
   [[nodiscard]] bool answer(std::optional<Error> refused);
+  /// For the run: who connects from now on waits for it. Between the two nobody was found there.
+  [[nodiscard]] std::unique_ptr<ControlListener> end() {
+    return ControlSocket::end(std::move(socket_));
+  }
 
  private:
   StartRoom(ServiceNotice& notice, hal::StopCategory declared)

@@ -4,13 +4,11 @@
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
 #include <utility>
 
 #include "apps/transport/control_path.hpp"
@@ -18,8 +16,6 @@
 namespace tandem::apps {
 namespace {
 
-constexpr mode_t kFolderMode = 0700;
-constexpr mode_t kSocketMode = 0600;
 /// A controller may have closed the descriptor that says so: the end is looked for, too.
 constexpr int kLookAround_ms = 500;
 
@@ -30,35 +26,6 @@ void wake(int eventfd) {
 
 std::string refused(const std::string& error, const std::string& hint) {
   return json_text({{"ok", false}, {"error", error}, {"hint", hint}});
-}
-
-std::string reason() { return std::strerror(errno); }
-
-/// The folder of the default paths is made when it is missing. Refused is one that others may
-/// change.
-Status prepare_folder(const std::string& path) {
-  const std::string folder = std::filesystem::path(path).parent_path().string();
-  if (folder != control_folder()) return check_socket_folder(path);
-  if (::mkdir(folder.c_str(), kFolderMode) != 0 && errno != EEXIST) {
-    return fail(fmt::format("cannot make the folder {}: {}", folder, reason()),
-                "choose another place with --socket");
-  }
-  return check_socket_folder(path);
-}
-
-/// Removes the socket of a dead process; what is anything else stays.
-Status clear_way(const std::string& path) {
-  struct stat found {};
-  if (::lstat(path.c_str(), &found) != 0) return {};
-  if (!S_ISSOCK(found.st_mode)) {
-    return fail(path + " is there, and no socket", "choose another place with --socket");
-  }
-  if (control_socket_alive(path)) {
-    return fail("another process listens at " + path, "choose another place with --socket");
-  }
-  if (::unlink(path.c_str()) == 0) return {};
-  return fail(fmt::format("cannot remove the stale socket {}: {}", path, reason()),
-              "remove it, or choose another place with --socket");
 }
 
 }  // namespace
@@ -81,71 +48,64 @@ struct ControlSocket::Client {
   bool gone = false;
 };
 
-ControlSocket::ControlSocket(std::string path, const ControlRegistry& registry)
-    : path_(std::move(path)), registry_(&registry) {}
+ControlSocket::ControlSocket(std::unique_ptr<ControlListener> listener,
+                             const ControlRegistry& registry)
+    : registry_(&registry), listener_(std::move(listener)) {}
 
 Result<std::unique_ptr<ControlSocket>> ControlSocket::open(const std::string& path,
                                                            const ControlRegistry& registry) {
-  std::unique_ptr<ControlSocket> socket(new ControlSocket(path, registry));
-  if (Status listening = socket->listen(); !listening) {
-    return std::unexpected(listening.error());
+  auto listener = ControlListener::open(path);
+  if (!listener) return std::unexpected(listener.error());
+  return open(std::move(*listener), registry);
+}
+
+Result<std::unique_ptr<ControlSocket>> ControlSocket::open(
+    std::unique_ptr<ControlListener> listener, const ControlRegistry& registry) {
+  std::unique_ptr<ControlSocket> socket(new ControlSocket(std::move(listener), registry));
+  socket->wake_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  socket->done_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  if (socket->wake_ < 0 || socket->done_ < 0) {
+    return fail(fmt::format("cannot serve {}: {}", socket->path(), std::strerror(errno)),
+                "close what has many files open");
   }
   socket->turns_ = std::make_unique<ControlTurns>(registry, [done = socket->done_] { wake(done); });
   socket->thread_ = std::thread([raw = socket.get()] { raw->serve(); });
   return socket;
 }
 
-Status ControlSocket::listen() {
-  const Result<sockaddr_un> address = control_address(path_);
-  if (!address) return std::unexpected(address.error());
-  if (Status ready = prepare_folder(path_); !ready) return ready;
-  if (Status clear = clear_way(path_); !clear) return clear;
-  listener_ = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  wake_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-  done_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-  struct stat made {};
-  // Nobody can connect before listen(), so the mode is right for the first who can.
-  const bool listens =
-      listener_ >= 0 && wake_ >= 0 && done_ >= 0 &&
-      ::bind(listener_, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) == 0 &&
-      ::chmod(path_.c_str(), kSocketMode) == 0 && ::stat(path_.c_str(), &made) == 0 &&
-      ::listen(listener_, SOMAXCONN) == 0;
-  if (!listens) {
-    return fail(fmt::format("cannot listen at {}: {}", path_, reason()),
-                "choose another place with --socket");
-  }
-  device_ = made.st_dev;
-  inode_ = made.st_ino;
-  return {};
-}
-
 ControlSocket::~ControlSocket() {
-  ending_ = true;
-  if (turns_ != nullptr) turns_->end();
-  wake(wake_);
-  if (thread_.joinable()) thread_.join();
-  if (turns_ != nullptr) {  // the run that a stop ends ends before the answer is out
-    for (std::size_t i = 0; i < kMaxControlClients && accept(); ++i) continue;
-    for (const auto& client : clients_) {
-      if (!client->waiting && client->out.empty()) take(*client);
-    }
-    turns_->finish();
-    deliver();
-  }
-  turns_.reset();
-  struct stat found {};
-  const bool ours = inode_ != 0 && ::lstat(path_.c_str(), &found) == 0 && found.st_dev == device_ &&
-                    found.st_ino == inode_;
-  if (ours) ::unlink(path_.c_str());
-  if (listener_ >= 0) ::close(listener_);
+  stop_serving(true);
   if (wake_ >= 0) ::close(wake_);
   if (done_ >= 0) ::close(done_);
+}
+
+std::unique_ptr<ControlListener> ControlSocket::end(std::unique_ptr<ControlSocket> socket) {
+  if (socket == nullptr) return nullptr;
+  socket->stop_serving(false);
+  return std::move(socket->listener_);
+}
+
+/// @param for_good  nobody serves after it: who waits to be accepted gets the last answers, too
+void ControlSocket::stop_serving(bool for_good) {
+  if (turns_ == nullptr) return;
+  ending_ = true;
+  turns_->end();
+  wake(wake_);
+  thread_.join();
+  // The run that a stop ends ends before the answer is out.
+  for (std::size_t i = 0; for_good && i < kMaxControlClients && accept(); ++i) continue;
+  for (const auto& client : clients_) {
+    if (!client->waiting && client->out.empty()) take(*client);
+  }
+  turns_->finish();
+  deliver();
+  turns_.reset();
 }
 
 void ControlSocket::serve() {
   std::vector<pollfd> watched;
   for (;;) {
-    watched.assign({{wake_, POLLIN, 0}, {done_, POLLIN, 0}, {listener_, POLLIN, 0}});
+    watched.assign({{wake_, POLLIN, 0}, {done_, POLLIN, 0}, {listener_->descriptor(), POLLIN, 0}});
     const std::size_t first = watched.size();
     for (const auto& client : clients_) {
       // A client with answers to come is not asked for more: it takes them first.
@@ -187,7 +147,7 @@ void ControlSocket::send_away(Client& client) {
 
 /// @return whether somebody waited
 bool ControlSocket::accept() {
-  const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+  const int fd = ::accept4(listener_->descriptor(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
   if (fd < 0) return false;
   // The socket's mode keeps others out already: this holds where a folder's or a copy's does not.
   if (const std::int64_t user = peer_user(fd); user != ::geteuid() && user != 0) {
@@ -290,9 +250,11 @@ void ControlSocket::flush(Client& client) {
 }
 
 Result<std::unique_ptr<ControlSocket>> serve(const ControlRegistry& registry,
-                                             const ControlSocketOptions& options) {
+                                             ControlSocketOptions options) {
   if (!options.wanted) return nullptr;
   const std::string& path = options.path;
+  if (options.listener != nullptr)
+    return ControlSocket::open(std::move(options.listener), registry);
   if (!path.empty()) {
     if (const Status ours = check_socket_folder(path); !ours) return std::unexpected(ours.error());
   }

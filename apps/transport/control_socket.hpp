@@ -2,8 +2,6 @@
 // Layer: apps/transport.  Thread: open/close main; one of its own talks, one for each turn answers.
 #pragma once
 
-#include <sys/types.h>
-
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -15,6 +13,7 @@
 
 #include "apps/control/control_registry.hpp"
 #include "apps/control/turns.hpp"
+#include "apps/transport/control_listener.hpp"
 #include "base/result.hpp"
 
 namespace tandem::apps {
@@ -36,25 +35,27 @@ static_assert(kMaxControlClients == 16);
 /// client has sent as it comes in, and parses kMaxUrgentQuestion bytes of a question at most.
 class ControlSocket {
  public:
-  /// Makes the folder of a default path (mode 0700) and the socket (mode 0600). The file of a dead
-  /// process is replaced.
   /// @param registry  complete; outlives the socket
-  /// Errors: a path that is too long; a folder that is missing, another user's or one that others
-  /// may change; a file that is
-  /// no socket; a process that listens there.
+  /// Errors: of ControlListener::open(); no descriptors are left.
   [[nodiscard]] static Result<std::unique_ptr<ControlSocket>> open(const std::string& path,
                                                                    const ControlRegistry& registry);
+  /// At the place of the one before: who waits there is served now.
+  [[nodiscard]] static Result<std::unique_ptr<ControlSocket>> open(
+      std::unique_ptr<ControlListener> listener, const ControlRegistry& registry);
+  /// Serves no more, and keeps the place: who connects from now on waits for who serves next.
+  /// @return the place; null of null
+  [[nodiscard]] static std::unique_ptr<ControlListener> end(std::unique_ptr<ControlSocket> socket);
   ~ControlSocket();
   ControlSocket(const ControlSocket&) = delete;
   ControlSocket& operator=(const ControlSocket&) = delete;
 
-  [[nodiscard]] const std::string& path() const noexcept { return path_; }
+  [[nodiscard]] const std::string& path() const noexcept { return listener_->path(); }
 
  private:
   struct Client;
-  ControlSocket(std::string path, const ControlRegistry& registry);
-  Status listen();
+  ControlSocket(std::unique_ptr<ControlListener> listener, const ControlRegistry& registry);
   void serve();
+  void stop_serving(bool for_good);
   bool accept();
   static void send_away(Client& client);
   void take(Client& client);
@@ -64,12 +65,9 @@ class ControlSocket {
   void drop_gone();
   void deliver();
 
-  std::string path_;
   const ControlRegistry* registry_;
-  int listener_ = -1;
-  int wake_ = -1;  // eventfd: the destructor's word to the thread
-  dev_t device_ = 0;
-  ino_t inode_ = 0;
+  std::unique_ptr<ControlListener> listener_;
+  int wake_ = -1;             // eventfd: the end's word to the thread
   std::uint64_t turn_ = 0;    // counts what clients do, to know who has been quiet
   std::uint64_t newest_ = 0;  // client's number
   std::vector<std::unique_ptr<Client>> clients_;
@@ -87,12 +85,13 @@ struct ControlSocketOptions {
   std::string kind;     ///< "run", "emulate"
   bool wanted = true;   ///< false: none is opened
   bool needed = false;  ///< a robot moves: without a way to stop it nothing starts
+  std::unique_ptr<ControlListener> listener{};  ///< of the one that served before, at `path`
 };
 
 /// Serves `registry`; null when no socket is wanted, or when it cannot be opened and is not needed,
 /// which is said on standard error. Errors: a socket that is needed, or whose path was named, and
 /// that cannot be opened; a path that was named in a folder that others may change.
 [[nodiscard]] Result<std::unique_ptr<ControlSocket>> serve(const ControlRegistry& registry,
-                                                           const ControlSocketOptions& options);
+                                                           ControlSocketOptions options);
 
 }  // namespace tandem::apps

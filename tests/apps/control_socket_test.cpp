@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <filesystem>
 #include <string>
 #include <thread>
 #include <vector>
@@ -266,6 +267,24 @@ TEST_F(Socket, AnswersAStopThatItsEndMeets) {
     EXPECT_EQ(line(fd), "{\"ok\":true,\"text\":\"stop\"}\n");
     ::close(fd);
   }
+}
+
+// A stop that came between the wait for a start and the run found nobody.
+TEST_F(Socket, IsAnsweredByWhoServesNext) {
+  auto listener = ControlSocket::end(open(path));
+  ASSERT_NE(listener, nullptr);
+  const int early = connect();
+  send(early, "{\"do\": \"echo\", \"text\": \"a\"}\n");
+  {
+    const auto next = ControlSocket::open(std::move(listener), registry);
+    ASSERT_TRUE(next.has_value());
+    EXPECT_EQ((*next)->path(), path);
+    EXPECT_EQ(line(early), "{\"ok\":true,\"text\":\"a\",\"times\":1}\n");
+    EXPECT_TRUE(ask(path, {{"do", "help"}}).has_value());
+  }
+  ::close(early);
+  EXPECT_FALSE(std::filesystem::exists(path));
+  EXPECT_EQ(ControlSocket::end(nullptr), nullptr);
 }
 
 // A run's studio closed before the thread of stops had answered.

@@ -1,9 +1,13 @@
-// What a reset is answered while the robot retreats, and when a fault follows it at once: the
-// commands of a run, its socket and `tandem fault reset`, over a robot of first order.
+// What a reset is answered while the robot retreats, and when a fault follows it at once, and a
+// stop that ends the run: its commands, its socket and `tandem fault reset`, over a robot of first
+// order.
 #include <unistd.h>
 
+#include <chrono>
+#include <future>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include "apps/clients/commands.hpp"
 #include "apps/control/run_control.hpp"
@@ -159,6 +163,37 @@ TEST_F(AnsweredRun, NamesTheCauseThatIsThereNow) {
   EXPECT_NE(err.find("7320"), std::string::npos) << err;
   EXPECT_EQ(err.find("8612"), std::string::npos) << err;
   EXPECT_EQ(registry.answer(R"({"do": "fault.show"})")["faults"].size(), 2U) << "told once";
+}
+
+/// Between the phase of the last cycle and what it confirms, it lets time pass.
+struct SlowEnd : hal::CycleObserver {
+  void take(const hal::CycleView& view) noexcept override {
+    if (view.phase == RunPhase::kDone) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+};
+
+// It was said that the run was over, and its loop stopped nothing any more: status 1, of a stop
+// that the loop was carrying out. The phase of its last cycle is seen before what that confirms.
+TEST(AnsweredStop, IsConfirmedByTheLastCycle) {
+  runtime::test::JointRun run;
+  SlowEnd slow;
+  run.observer = &slow;
+  run.backend.shut_down_cycles = 2;
+  run.begin({});
+  ControlRegistry registry;
+  add_run_commands(registry, *run.cycle, run.robot);
+  run.cycle->inbox().end_run();
+  run.steps(1);
+  ASSERT_EQ(run.cycle->phase(), RunPhase::kShutDown);
+  auto answer =
+      std::async(std::launch::async, [&] { return registry.answer(R"({"do": "estop"})"); });
+  while (!run.cycle->inbox().is_urgent()) std::this_thread::yield();
+  EXPECT_FALSE(run.cycle->step());
+  EXPECT_EQ(run.cycle->phase(), RunPhase::kDone);
+  const Json confirmed = answer.get();
+  EXPECT_EQ(confirmed.value("confirmed", false), true) << confirmed;
+  const Json late = registry.answer(R"({"do": "estop"})");
+  EXPECT_EQ(late.value("error", ""), "the run is over: its loop stops nothing any more") << late;
 }
 
 }  // namespace
