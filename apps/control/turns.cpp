@@ -1,14 +1,18 @@
 #include "apps/control/turns.hpp"
 
 #include <algorithm>
+#include <system_error>
 #include <utility>
 
 namespace tandem::apps {
 
 ControlTurns::ControlTurns(const ControlRegistry& registry, std::function<void()> answered)
     : registry_(&registry), answered_(std::move(answered)) {
-  for (Turn& turn : turns_) {
-    turn.thread = std::thread([this, &turn] { work(turn); });
+  try {
+    for (Turn& turn : turns_) turn.thread = std::thread([this, &turn] { work(turn); });
+  } catch (const std::system_error&) {  // no more threads: the first ones end, and are waited for
+    finish();
+    throw;
   }
 }
 

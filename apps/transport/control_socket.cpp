@@ -91,7 +91,7 @@ void ControlSocket::stop_serving(bool for_good) {
   ending_ = true;
   turns_->end();
   wake(wake_);
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
   // The run that a stop ends ends before the answer is out.
   for (std::size_t i = 0; for_good && i < kMaxControlClients && accept(); ++i) continue;
   for (const auto& client : clients_) {

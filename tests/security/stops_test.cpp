@@ -26,6 +26,7 @@
 #include "tests/support/dds_domain.hpp"
 #include "tests/support/eventually.hpp"
 #include "tests/support/needs_root.hpp"
+#include "tests/support/socket_path.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -330,7 +331,8 @@ TEST_F(StopUnderAttack, AControllerThatClosesEveryDescriptorIsEnded) {
 }
 
 /// Runs `tandem ARGUMENTS` as a user who runs nothing else, with so many threads.
-int run_with_threads(const std::filesystem::path& folder, rlim_t most,
+/// @param sockets  where nothing is, or that user's folder
+int run_with_threads(const std::filesystem::path& folder, rlim_t most, const std::string& sockets,
                      const std::string& arguments) {
   const uid_t user = 40'000 + static_cast<uid_t>(::getpid() % 20'000);
   const pid_t child = ::fork();
@@ -343,6 +345,7 @@ int run_with_threads(const std::filesystem::path& folder, rlim_t most,
         ::setrlimit(RLIMIT_NPROC, &limit) != 0) {
       ::_exit(99);
     }
+    ::setenv("TANDEM_SOCKETS", sockets.c_str(), 1);
     const std::string program = shell_word(TANDEM_BINARY_DIR "/bin/tandem");
     ::execl("/bin/sh", "sh", "-c", ("exec " + program + " " + arguments).c_str(), nullptr);
     ::_exit(98);
@@ -352,30 +355,32 @@ int run_with_threads(const std::filesystem::path& folder, rlim_t most,
   return WIFEXITED(raw) ? WEXITSTATUS(raw) : 128 + WTERMSIG(raw);
 }
 
-// It ended by abort(), with status 134.
+// It ended by abort(), with status 134; and later still did where it has a socket.
 TEST_F(StopUnderAttack, ARunThatGetsNoThreadsSaysWhatToDo) {
   if (::geteuid() != 0) GTEST_SKIP() << test::needs_root("a user who has no other processes");
   std::filesystem::permissions(folder_, std::filesystem::perms::all);
-  if (run_with_threads(folder_, 1000, "--version") != 0) {
+  const std::string sockets = test::socket_path("-threads");
+  if (run_with_threads(folder_, 1000, sockets, "--version") != 0) {
     GTEST_SKIP() << "another user cannot run this build: a folder above it is closed";
   }
   int refused = 0, done = 0;
-  for (const char* dds : {"", " --dds"}) {
+  for (const std::string& doors :
+       {std::string(" --no-socket"), " --no-socket --dds" + domain(), std::string()}) {
     for (rlim_t most = 1; most < 40; ++most) {
-      SCOPED_TRACE(fmt::format("{} threads{}", most, dds));
-      const int status =
-          run_with_threads(folder_, most,
-                           "run hold.toml --no-log -q --duration 0.1 --no-build --no-socket" +
-                               std::string(dds) + (*dds == '\0' ? "" : domain()));
+      SCOPED_TRACE(fmt::format("{} threads{}", most, doors));
+      const int status = run_with_threads(
+          folder_, most, sockets, "run hold.toml --no-log -q --duration 0.1 --no-build" + doors);
       const std::string told = read_text(folder_ / "threads.txt");
       EXPECT_TRUE(status == 0 || status == 2) << status << ": " << told;
       EXPECT_TRUE(status == 0 || has(told, "threads")) << told;
+      EXPECT_FALSE(has(told, "no control socket")) << told;
       ++(status == 0 ? done : refused);
       if (status == 0) break;
     }
   }
   EXPECT_GT(refused, 3);
-  EXPECT_EQ(done, 2);
+  EXPECT_EQ(done, 3);
+  std::filesystem::remove_all(sockets);
 }
 
 // Whose ports.
