@@ -450,6 +450,7 @@ std::optional<Exit> reach(WiredComposition& c, const RunOptions& options, Servic
 /// @param again  why it waits for its start again; set where it is to do so once more
 Exit run_once(RunOptions options, Gate* gate, ServiceNotice& notice, ReportOfRun& report,
               StartRoom::Before& again) {
+  StartRoom::Before before = std::exchange(again, {});
   auto composition = runtime::composed<WiredComposition>(
       options.experiment, options,
       {.build = options.lacks_kernels.empty() ? builder(options.quiet)
@@ -463,7 +464,7 @@ Exit run_once(RunOptions options, Gate* gate, ServiceNotice& notice, ReportOfRun
   if (const Diagnostics errors = check_events((*composition)->experiment); !errors.empty())
     return refuse(errors);
   std::unique_ptr<ControlListener> listens;
-  if (const auto ended = reach(**composition, options, notice, std::exchange(again, {}), listens))
+  if (const auto ended = reach(**composition, options, notice, std::move(before), listens))
     return *ended;
   print_warnings((*composition)->warnings);
   set_pace(**composition, options);

@@ -241,6 +241,20 @@ TEST_F(Service, WaitsAgainWhereNoDriveCouldBeEnabled) {
   EXPECT_EQ(end(), 0) << said();
 }
 
+// It read them again and again, and never ended.
+TEST_F(Service, EndsWhereItsFilesAreWrongWhenItWaitsAgain) {
+  write_text(folder_ / "dead.toml",
+             read_text(folder_ / "hold.toml") +
+                 "\n[[fault]]\nkind = \"board_kill\"\nboard = \"board_1\"\nat_s = 0\n");
+  begin("--rate 20 --duration endless --wait-for-start", "dead.toml", "60000000");
+  ASSERT_TRUE(manager_.hears("READY=1"));
+  write_text(folder_ / "dead.toml", "nonsense = 1\n");
+  EXPECT_EQ(to_run("controller start").status, 0);
+  EXPECT_EQ(end(), 2);
+  EXPECT_NE(said().find("nonsense"), std::string::npos) << said();
+  EXPECT_EQ(said().find("nonsense"), said().rfind("nonsense")) << "said once";
+}
+
 // The service of a robot that had booted ended with its start, and nobody could start it again but
 // root.
 TEST_F(Service, WaitsOnWhereTheDiskHasNoRoomForItsLog) {
