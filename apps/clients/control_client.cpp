@@ -113,8 +113,7 @@ Error ended() {
   return {.message = kEnded, .hint = "its own output and its log say how", .file = {}, .key = {}};
 }
 
-/// Whether a socket is there again within a second: a process that waited for its start has one for
-/// the wait and then one for the run.
+/// Whether a socket is there again within a second: of a run that begins where another one ended.
 bool comes_back(const std::string& path) {
   for (int tries = 0; has_ended(path); ++tries) {
     if (tries == 20) return false;

@@ -27,12 +27,12 @@ inline constexpr std::size_t kMaxControlClients = 16;
 inline constexpr char kTooManyClients[] = "16 clients are there already";
 static_assert(kMaxControlClients == 16);
 
-/// Serves a registry until it is destroyed; the file is removed then. Nothing that a client does
-/// or leaves undone reaches the process: a client that sends a line that is too long, that does
-/// not read its answers, or that is gone, is closed. What such a client asked for and has not begun
-/// is dropped, unless it stops the robot. A client's questions are answered in order; one whose
-/// turn is urgent waits for no other client's: who talks answers nothing itself, reads what a new
-/// client has sent as it comes in, and parses kMaxUrgentQuestion bytes of a question at most.
+/// Serves a registry until it is destroyed, and the file with it, or until end(). Nothing that a
+/// client does or leaves undone reaches the process: a client that sends a line that is too long,
+/// that does not read its answers, or that is gone, is closed. What such a client asked for and has
+/// not begun is dropped, unless it stops the robot. A client's questions are answered in order; one
+/// whose turn is urgent waits for no other client's: who talks answers nothing itself, reads what a
+/// new client has sent as it comes in, and parses kMaxUrgentQuestion bytes of a question at most.
 class ControlSocket {
  public:
   /// @param registry  complete; outlives the socket

@@ -26,6 +26,13 @@ class Service : public Program {
     ::unsetenv("NOTIFY_SOCKET");
     ::unsetenv("WATCHDOG_USEC");
   }
+  /// A run of dead.toml that waits for its start, and none of whose drives can be enabled.
+  void begin_without_power() {
+    write_text(folder_ / "dead.toml",
+               read_text(folder_ / "hold.toml") +
+                   "\n[[fault]]\nkind = \"board_kill\"\nboard = \"board_1\"\nat_s = 0\n");
+    begin("--rate 20 --duration endless --wait-for-start", "dead.toml", "60000000");
+  }
   [[nodiscard]] Outcome to_run(const std::string& command) const {
     return tandem(command + " --socket " + socket_);
   }
@@ -226,10 +233,7 @@ TEST_F(Service, WaitsOnForARobotThatIsNotThere) {
 
 // Its drives had no power: the service of a fresh robot ended after ten seconds.
 TEST_F(Service, WaitsAgainWhereNoDriveCouldBeEnabled) {
-  write_text(folder_ / "dead.toml",
-             read_text(folder_ / "hold.toml") +
-                 "\n[[fault]]\nkind = \"board_kill\"\nboard = \"board_1\"\nat_s = 0\n");
-  begin("--rate 20 --duration endless --wait-for-start", "dead.toml", "60000000");
+  begin_without_power();
   ASSERT_TRUE(manager_.hears("READY=1"));
   EXPECT_EQ(to_run("controller start").status, 0);
   EXPECT_TRUE(
@@ -243,10 +247,7 @@ TEST_F(Service, WaitsAgainWhereNoDriveCouldBeEnabled) {
 
 // It read them again and again, and never ended.
 TEST_F(Service, EndsWhereItsFilesAreWrongWhenItWaitsAgain) {
-  write_text(folder_ / "dead.toml",
-             read_text(folder_ / "hold.toml") +
-                 "\n[[fault]]\nkind = \"board_kill\"\nboard = \"board_1\"\nat_s = 0\n");
-  begin("--rate 20 --duration endless --wait-for-start", "dead.toml", "60000000");
+  begin_without_power();
   ASSERT_TRUE(manager_.hears("READY=1"));
   write_text(folder_ / "dead.toml", "nonsense = 1\n");
   EXPECT_EQ(to_run("controller start").status, 0);
